@@ -47,7 +47,7 @@ def test_a_tuner_keeps_to_every_budget_that_a_spec_permits(name: str, options: A
     for evaluations in {max(2, ensemble), ensemble + 1, 2 * ensemble + 1, 30, 61}:
         physics = Physics()
 
-        found = tuned(lambda: tuner(name, options), physics, ensemble, evaluations=evaluations)  # type: ignore[arg-type]
+        found = tuned(tuner(name, options), physics, ensemble, evaluations=evaluations)
 
         assert physics.rollouts <= evaluations * 3
         assert len(found) == ensemble
@@ -85,7 +85,7 @@ def test_rounds_are_fewer_where_the_budget_has_too_few_evaluations() -> None:
     for evaluations, sizes in ((60, [2] * 30), (61, [2] * 30), (3, [3]), (2, [2])):
         physics = Physics()
 
-        tuned(lambda: tuner("abc_smc", {"rounds": 100}), physics, evaluations=evaluations)  # type: ignore[arg-type]
+        tuned(tuner("abc_smc", {"rounds": 100}), physics, evaluations=evaluations)
 
         assert [len(asked) for asked in physics.asked] == sizes
 
