@@ -48,7 +48,8 @@ class EstimationExploration(Strategy):
     """Competing models of the robot, and tests that are fit, or that tell the models apart.
 
     A test should make the models disagree, but not a model with itself after a slight change of its tunables. For the
-    authors' estimation, combine it with the tuner `climbers` and the discrepancy `readings`.
+    authors' estimation, combine it with the tuner `climbers` and the discrepancy `readings`. Do not select by
+    disagreement where impacts are chaotic: models disagree most on what none of them can predict.
     """
 
     name = "estimation_exploration"
