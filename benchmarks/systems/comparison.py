@@ -40,6 +40,7 @@ TITLES = {
     "outside": "outside",
     "outside-noisy": "outside with noise",
 }
+NEITHER = "- No pair of systems is shown in both directions. Where leaders change above, chance may have chosen them."
 WIDTH_IN = 9.0
 HEIGHT = 4.6
 """Of a panel, as a factor of the usual height: each system has a line of text."""
@@ -216,12 +217,14 @@ def _where(key: tuple[str, str, Fitness]) -> str:
 def page(found: Columns) -> str:
     """Return the document."""
     text = (Path(__file__).parent / "comparison.txt").read_text("utf-8")
-    turned = "\n".join(f"- {line}" for line in reversals(found)) or "- No pair of systems is shown in both directions."
+    turned = "\n".join(f"- {line}" for line in reversals(found)) or NEITHER
     left = [title for reality, title in TITLES.items() if reality not in _realities(found)]
     missing = f"\nNot computed: {listed(left)}.\n" if left else ""
     return text.format(
         table=rows(found),
         answers=answers(found),
+        last=leaders(found, "ten evaluations", Fitness.TRANSFERRED)[-1],
+        kept=leaders(found, "ten evaluations", Fitness.EQUAL_CHANCES)[-1],
         undecided=undecided(found),
         systems=len(_systems()),
         reversals=turned,
@@ -230,24 +233,19 @@ def page(found: Columns) -> str:
 
 
 def answers(found: Columns) -> str:
-    """Return which system has the best mean: a row for what is equal and whose fitness counts, a column for a reality.
-
-    The last column is the best average over the realities, of the systems that are in each of them.
-    """
-    lines = []
-    for equal in EQUAL:
-        for kind in KINDS:
-            ones = [found[each, equal, kind] for each in _realities(found)]
-            means = [{place: cell.mean for place, cell in one.cells.items() if place in _systems()} for one in ones]
-            everywhere = set.intersection(*map(set, means))
-            average = {place: sum(each[place] for each in means) / len(means) for place in everywhere}
-            lines.append([f"{equal}, {IN_SHORT[kind]}", *map(_leader, means), _leader(average)])
+    """Return which system leads: a row for what is equal and whose fitness counts, a column for a reality."""
+    lines = [[f"{equal}, {words}", *leaders(found, equal, kind)] for equal in EQUAL for kind, words in IN_SHORT.items()]
     return table(["equal", *(TITLES[each] for each in _realities(found)), "on average"], lines)
 
 
-def _leader(means: Mapping[int, float]) -> str:
-    best = max(means, key=lambda place: means[place])
-    return f"{ROWS[best].name} {100 * means[best]:.0f}"
+def leaders(found: Columns, equal: str, kind: Fitness) -> list[str]:
+    """Return the system with the best mean in each reality, and on average of those that are in every reality."""
+    ones = [found[each, equal, kind] for each in _realities(found)]
+    means = [{place: cell.mean for place, cell in one.cells.items() if place in _systems()} for one in ones]
+    everywhere = set.intersection(*map(set, means))
+    means.append({place: sum(each[place] for each in means) / len(means) for place in everywhere})
+    best = [max((mean, place) for place, mean in each.items()) for each in means]
+    return [f"{ROWS[place].name} {100 * mean:.0f}" for mean, place in best]
 
 
 def undecided(found: Columns) -> str:
