@@ -135,20 +135,19 @@ def _within(pairs: Sequence[Comparison]) -> str:
 
 
 def _disagreements(pairs: Sequence[Comparison], names: Mapping[str, str]) -> Iterator[str]:
-    """Yield the pairs on which other tests of the same kind, unpaired or paired, disagree with the trusted one."""
+    """Yield on which pairs other tests of the same kind, unpaired or paired, disagree with the trusted one."""
+    alike: dict[str, list[str]] = {}
     for pair in pairs:
         unpaired = {"Student's t": pair.student, "Mann-Whitney": pair.mann_whitney}
         tests = {"Wilcoxon": pair.wilcoxon} if pair.shared_streams else unpaired
         known = {name: test for name, test in tests.items() if test.p_holm is not None}
         other = [name for name, test in known.items() if test.differs != pair.differs]
         if other and pair.trusted.p_holm is not None:
-            found, p = (
-                ("differ", f"p of at least {SIGNIFICANT}")
-                if pair.differs
-                else ("are not shown to differ", f"p below {SIGNIFICANT}")
-            )
-            both = f"{names[pair.first]} and {names[pair.second]}"
-            yield f"{both} {found} by the test that the verdict uses, although {listed(other)} has a {p}."
+            found, p = ("differ", "at least") if pair.differs else ("are not shown to differ", "below")
+            told = f"{found} by the test that the verdict uses, although p is {p} {SIGNIFICANT} by {listed(other)}"
+            alike.setdefault(told, []).append(f"{names[pair.first]} and {names[pair.second]}")
+    for told, both in alike.items():
+        yield f"Pairs that {told}: {'; '.join(both)}."
 
 
 def share_of_direct(learned: Sequence[Judged], judged: Sequence[Judged], pairs: Sequence[Comparison]) -> Iterator[str]:
@@ -185,7 +184,7 @@ def end_of_curve(one: Judged, end: CurveEnd) -> str:
     """Return the trend at the end of a curve in words, with its numbers."""
     if end.trend is Trend.TOO_FEW or end.gain is None:
         counts = f"{number_of('repetition', end.n)} at {evaluations(end.last, one.curve.known)}"
-        return f"{one.name}: {counts} are too few to say whether it still rises."
+        return f"{one.name}: {counts} are too few to say whether fitness still rises."
     gain = f"{signed(end.gain)} {one.curve.unit}, {interval(end.lower, end.upper, signed)}"
     words = {
         Trend.RISING: "still rises; continuing is worthwhile",
@@ -194,6 +193,15 @@ def end_of_curve(one: Judged, end: CurveEnd) -> str:
         Trend.UNCLEAR: "may still rise or not; more repetitions would tell",
     }[end.trend]
     return f"{one.name} {words} (gain from {end.since} to {end.last} evaluations: {gain})."
+
+
+def _endings(trends: Sequence[TrendRead]) -> Iterator[str]:
+    """Yield how curves end, those that end alike in one sentence."""
+    alike: dict[str, list[str]] = {}
+    for trend in trends:
+        alike.setdefault(trend.sentence.removeprefix(trend.name), []).append(trend.name)
+    for end, names in alike.items():
+        yield f"{listed(names)}{end}"
 
 
 def continuing(trends: Sequence[TrendRead]) -> Iterator[str]:
@@ -281,7 +289,7 @@ def judge(
     told = [
         *ranking(learned, pairs, names, after),
         *share_of_direct(learned, judged, pairs),
-        *(trend.sentence for trend in trends),
+        *_endings(trends),
         *spread(learned),
         *incomplete(experiments, names),
     ]

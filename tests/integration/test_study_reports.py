@@ -159,6 +159,26 @@ def test_the_verdict_on_two_strategies(sqlite_store: Store, ahead: float, headli
     assert verdict.headline.replace("\xa0", " ").startswith(headline)
 
 
+def test_the_verdict_says_once_what_holds_of_several(sqlite_store: Store) -> None:
+    spec = toy(iterations=2, repetitions=8).model_dump(mode="json", exclude_unset=True, exclude={"strategy"})
+    strategies = ["random", "known_fit", "farthest"]
+    made = submission.submit(sqlite_store, StudySpec.model_validate({**spec, "strategies": strategies}))
+    worse = made.experiments[1].id
+    for claim in execution.claim(sqlite_store, "test", limit=24):
+        last = 1.0 if claim.experiment_id != worse else 0.5 if claim.number else 20.0
+        record(sqlite_store, claim, [0.1, 0.2, last], spread=0.02)
+
+    verdict = verdict_on(sqlite_store, reading.read(sqlite_store, made.id))
+    told = [sentence.replace("\xa0", " ") for sentence in verdict.sentences]
+
+    assert (
+        "Pairs that are not shown to differ by the test that the verdict uses, although p is below 0.05 by "
+        "Mann-Whitney: Random and Known fit; Known fit and Farthest." in told
+    )
+    few = "8 repetitions at 2 real-world evaluations are too few to say whether fitness still rises."
+    assert f"Random, Known fit and Farthest: {few}" in told
+
+
 def test_the_verdict_tells_the_share_of_direct(published: Store, study: str) -> None:
     sentences = verdict_on(published, reading.read(published, study)).sentences
 
