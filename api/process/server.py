@@ -4,6 +4,9 @@ import signal
 import socket
 import sys
 from asyncio import TimerHandle, Transport
+from collections.abc import Generator
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 import h11
@@ -207,6 +210,13 @@ class Server(uvicorn.Server):
         super().__init__(config)
         self._app = app
 
+    @contextmanager
+    def capture_signals(self) -> Generator[None, None, None]:
+        """Take signals from now on; one that came before, and whose exception was lost, counts too."""
+        with super().capture_signals():
+            self.should_exit = self.should_exit or bool(_came)
+            yield
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End the streams and the replay process, finish the requests under way, and close."""
         self._app.state.feed.close()
@@ -214,9 +224,21 @@ class Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
+_came: list[int] = []
+"""Signals so far that were turned into SystemExit."""
+
+
 def exit_on_signals() -> None:
-    """Turn SIGINT and SIGTERM into SystemExit, so that `finally` blocks close what is open; a lost terminal too."""
+    """Turn SIGINT and SIGTERM into SystemExit, so that `finally` blocks close what is open; a lost terminal too.
+
+    Python drops an exception that is raised while it frees an object, so a `Server` asks which signals came.
+    """
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: sys.exit(0))
+        signal.signal(number, _leave)
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as `nohup` sets it
         signal.signal(signal.SIGHUP, lambda *_: signal.raise_signal(signal.SIGTERM))
+
+
+def _leave(number: int, _: FrameType | None) -> None:
+    _came.append(number)
+    sys.exit(0)

@@ -42,6 +42,16 @@ def alive(pid: int) -> bool:
         return False
 
 
+FREED = """
+from signal import SIGTERM, raise_signal
+
+class Freed:
+    def __del__(self):
+        raise_signal(SIGTERM)
+
+Freed()
+"""
+
 LINGERING = "from threading import Event, Thread\n\nThread(target=Event().wait).start()\n"
 
 
@@ -69,6 +79,18 @@ def ended(environment: dict[str, str], *arguments: str) -> tuple[int, str]:
 @pytest.fixture
 def port() -> int:
     return free_port()
+
+
+def test_a_signal_that_comes_while_python_frees_an_object_ends_the_service(
+    tmp_path: Path, sqlite_url: str, port: int
+) -> None:
+    (tmp_path / "freed.py").write_text(FREED)
+    environment = {"GAPLAB_DATABASE_URL": sqlite_url, "GAPLAB_PLUGINS": str(tmp_path), "GAPLAB_PORT": str(port)}
+
+    code, said = ended(environment, "--no-workers")
+
+    assert "Exception ignored" in said
+    assert code == 0
 
 
 @pytest.mark.parametrize(
